@@ -151,8 +151,8 @@ def text_table(path: Path) -> Table:
         raise ScenarioError(f"{path}: is empty")
     if not told and (left := before(lines, path)):
         table.notes.append(
-            f"{left} lines before the head of the table are left out ({lines[0].strip()[:40]!r} "
-            f"first); its head is {lines[left].strip()[:60]!r}"
+            f"what stands before the head of the table is left out ({left} lines, the first "
+            f"{lines[0].strip()[:40]!r}); its head is {lines[left].strip()[:60]!r}"
         )
         lines = lines[left:]
     separator = told["separator"] if told else separator_of(lines)

@@ -74,7 +74,7 @@ def integer_of(element: ET.Element, key: str) -> int:
     Raises:
         Unsound: it is missing, or none.
     """
-    return _read(element, key, needed(element, key), whole_of)
+    return _read(element, key, needed(element, key), _whole_of)
 
 
 def wholes_of(element: ET.Element, key: str) -> list[int]:
@@ -83,7 +83,7 @@ def wholes_of(element: ET.Element, key: str) -> list[int]:
     Raises:
         Unsound: one is none.
     """
-    return [_read(element, key, item, whole_of) for item in element.get(key, "").split()]
+    return [_read(element, key, item, _whole_of) for item in element.get(key, "").split()]
 
 
 def number_of(element: ET.Element, key: str) -> float | None:
@@ -93,7 +93,7 @@ def number_of(element: ET.Element, key: str) -> float | None:
         Unsound: it is no number.
     """
     text = element.get(key)
-    return None if text is None else _read(element, key, text, float_of)
+    return None if text is None else _read(element, key, text, _float_of)
 
 
 def _read(element: ET.Element, key: str, text: str, reader: Callable[[str], Scalar]) -> Scalar:
@@ -103,24 +103,16 @@ def _read(element: ET.Element, key: str, text: str, reader: Callable[[str], Scal
         raise Unsound(f"{named(element)} has {key} = {shown(text)}, {error}") from None
 
 
-def whole_of(text: str) -> int:
-    """A whole number as XML writes it.
-
-    Raises:
-        ValueError: it is none; the text says so.
-    """
+def _whole_of(text: str) -> int:
+    """A whole number as XML writes it."""
     try:
         return int("" if "_" in text else text)  # Python takes 1_000 for a number
     except ValueError:
         raise ValueError("which is no whole number") from None
 
 
-def float_of(text: str) -> float:
-    """A number as XML writes it.
-
-    Raises:
-        ValueError: it is none; the text says so.
-    """
+def _float_of(text: str) -> float:
+    """A number as XML writes it."""
     try:
         return float("" if "_" in text else text)
     except ValueError:
@@ -196,11 +188,11 @@ def start_of(element: ET.Element, type_: str, key: str = "start") -> tuple[Start
         return (text,)
     if type_ == "Binary":
         return (_read(element, key, text, _bytes_of),)
-    reader: Callable[[str], Any] = float_of
+    reader: Callable[[str], Any] = _float_of
     if type_.startswith("Boolean"):
         reader = _truth_of
     elif type_ in INTEGERS:
-        reader = whole_of
+        reader = _whole_of
     return tuple(_read(element, key, item, reader) for item in text.split())
 
 
@@ -221,7 +213,7 @@ class Types:
     def number(self, element: ET.Element, key: str) -> float | None:
         """The same of a floating-point attribute."""
         text = self.get(element, key)
-        return None if text is None else _read(element, key, text, float_of)
+        return None if text is None else _read(element, key, text, _float_of)
 
     def items(self, element: ET.Element) -> dict[int, str]:
         """Names of the values of an enumeration; FMI 2 counts from 1 where it does not say."""

@@ -7,7 +7,7 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from ..reading.limits import VALUES
 from ..spec.units import Unit
@@ -131,13 +131,44 @@ def read_variables(
     return variables
 
 
-def _kind(element: ET.Element, continuous: bool) -> tuple[str, str, str]:
-    """Causality, variability and initial, with FMI's defaults filled in."""
+def _variable(
+    element: ET.Element,
+    inner: ET.Element,
+    type_: str,
+    types: Types,
+    units: Mapping[str, Unit],
+    **more: Any,
+) -> Variable:
+    """A variable, with FMI's defaults filled in.
+
+    Args:
+        element: that says what it is.
+        inner: that says what its type is; of FMI 3 the same.
+        type_: its name here.
+        types: that are declared.
+        units: that are declared.
+        more: its other attributes.
+    """
     causality = one_of(element, "causality", get_args(Causality), "local")
-    default = "continuous" if continuous else "discrete"
+    default = "continuous" if type_ in ("Float64", "Float32") else "discrete"
     variability = one_of(element, "variability", VARIABILITIES, default)
     given = one_of(element, "initial", INITIALS, "")
-    return causality, variability, initial_of(given, causality, variability)
+    return Variable(
+        name=needed(element, "name"),
+        reference=integer_of(element, "valueReference"),
+        type=type_,
+        causality=causality,
+        variability=variability,
+        initial=initial_of(given, causality, variability),
+        unit=unit_of(types.get(inner, "unit"), units),
+        minimum=types.number(inner, "min"),
+        maximum=types.number(inner, "max"),
+        nominal=types.number(inner, "nominal"),
+        text=element.get("description", ""),
+        relative=types.get(inner, "relativeQuantity") in _TRUE,
+        items=types.items(inner) if type_.startswith("Enumeration") else None,
+        **more,
+    )
 
 
 def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
@@ -148,25 +179,8 @@ def _variables2(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
         if inner is None:
             raise Unsound(f"{named(element)} has no type ({', '.join(FMI2_TYPES)})")
         type_ = FMI2_TYPES[inner.tag]
-        causality, variability, initial = _kind(element, inner.tag == "Real")
-        found.append(
-            Variable(
-                name=needed(element, "name"),
-                reference=integer_of(element, "valueReference"),
-                type=type_,
-                causality=causality,
-                variability=variability,
-                initial=initial,
-                unit=unit_of(types.get(inner, "unit"), units),
-                start=start_of(inner, type_),
-                minimum=types.number(inner, "min"),
-                maximum=types.number(inner, "max"),
-                nominal=types.number(inner, "nominal"),
-                text=element.get("description", ""),
-                relative=inner.tag == "Real" and types.get(inner, "relativeQuantity") in _TRUE,
-                items=types.items(inner) if inner.tag == "Enumeration" else None,
-            )
-        )
+        start = start_of(inner, type_)
+        found.append(_variable(element, inner, type_, types, units, start=start))
     return found
 
 
@@ -220,27 +234,9 @@ def _variables3(root: ET.Element, units: Mapping[str, Unit]) -> list[Variable]:
         )
         if dimensions and len(start) == 1:
             start = start * math.prod(dimensions)
-        causality, variability, initial = _kind(element, type_ in ("Float64", "Float32"))
-        found.append(
-            Variable(
-                name=needed(element, "name"),
-                reference=integer_of(element, "valueReference"),
-                type=type_,
-                causality=causality,
-                variability=variability,
-                initial=initial,
-                unit=unit_of(types.get(element, "unit"), units),
-                start=start,
-                minimum=types.number(element, "min"),
-                maximum=types.number(element, "max"),
-                nominal=types.number(element, "nominal"),
-                text=element.get("description", ""),
-                dimensions=dimensions,
-                relative=types.get(element, "relativeQuantity") in _TRUE,
-                intermediate=element.get("intermediateUpdate") in _TRUE,
-                items=types.items(element) if type_ == "Enumeration" else None,
-            )
-        )
+        intermediate = element.get("intermediateUpdate") in _TRUE
+        more = {"start": start, "dimensions": dimensions, "intermediate": intermediate}
+        found.append(_variable(element, element, type_, types, units, **more))
         found += [
             replace(
                 found[-1],

@@ -125,7 +125,7 @@ def test_lines_before_the_head_are_left_out(tmp_path: Path, before: str, units: 
     assert found["y"] == pytest.approx(2.0 * np.arange(20), abs=0.0)
     assert found.units["u"] == ("V" if units else "")
     left = len([line for line in before.splitlines() if line.strip()])
-    assert f"{left} lines before the head of the table are left out" in found.notes[0]
+    assert f"before the head of the table is left out ({left} lines" in found.notes[0]
 
 
 @pytest.mark.parametrize(
