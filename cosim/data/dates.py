@@ -2,6 +2,7 @@
 
 2025-03-01T10:00:00.020Z    since 1970; without a zone UTC is taken
 10:00:00.020                since midnight; a step back by more than half a day is the next one
+2025-03-01, 10:00:00.020    a column of dates beside one of times of day: one clock, as the first
 stamp.secs, stamp.nsecs     one clock `stamp`, as messages of ROS have it in two parts
 """
 
@@ -22,6 +23,7 @@ _MOMENT = re.compile(
 )
 """ISO 8601, with a blank for its T, and with slashes, as long as the year comes first."""
 _OF_DAY = re.compile(r"(?P<time>\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?)")
+_DATE = re.compile(r"\d{4}[-/]\d\d[-/]\d\d")
 YEARS = (1678, 2261)
 """Whole ones that 64 bits of nanoseconds since 1970 reach."""
 _LIKE = re.compile(
@@ -44,7 +46,7 @@ def nanoseconds(cells: Sequence[str]) -> tuple[list[int | None], str] | None:
 
     Every cell must be one, but for those that say that they are missing.
     """
-    texts = [cell.strip().strip('"').strip() for cell in cells]
+    texts = [_bare(cell) for cell in cells]
     said = [text for text in texts if text.lower() not in MISSING]
     if not said:
         return None
@@ -104,6 +106,32 @@ def _of_day(found: list[re.Match[str]]) -> tuple[list[int], str]:
             days += 1
         counts.append(count + days * 2 * _HALF_DAY)
     return counts, "times of day, counted in ns since midnight"
+
+
+def beside(columns: Mapping[str, Sequence[str]]) -> tuple[str, str, list[str]] | None:
+    """Dates and times of day in two columns: names of both, and their cells as moments.
+
+    None unless there is one column of each; a row lacks its moment if it lacks one of both.
+    """
+    days = [name for name, cells in columns.items() if _all(_DATE, cells)]
+    times = [name for name, cells in columns.items() if _all(_OF_DAY, cells)]
+    if len(days) != 1 or len(times) != 1:
+        return None
+    both = [
+        "" if {day.lower(), time.lower()} & MISSING else f"{day} {'0' * (time[1] == ':')}{time}"
+        for day, time in zip(*(map(_bare, columns[n]) for n in (*days, *times)), strict=True)
+    ]
+    return days[0], times[0], both
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().strip('"').strip()
+
+
+def _all(pattern: re.Pattern[str], cells: Sequence[str]) -> bool:
+    """Whether cells are of a pattern, but for those that say that they are missing."""
+    said = [text for text in map(_bare, cells) if text.lower() not in MISSING]
+    return bool(said) and all(map(pattern.fullmatch, said))
 
 
 def in_two_parts(columns: Mapping[str, Vector]) -> dict[str, tuple[str, list[int]]]:

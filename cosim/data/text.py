@@ -184,12 +184,17 @@ def text_table(path: Path) -> Table:
         name: [row[index] if index < len(row) else "" for row in rows]
         for index, (name, _) in enumerate(names)
     }
+    told_units = dict(zip(columns, units, strict=True))
+    if moments := dates.beside(columns):
+        day, time, columns[time] = moments
+        del columns[day]
+        table.notes.append(f"columns {day!r} and {time!r} are one clock {time!r}")
     commas = {
         name: decimal_comma(cells)
         for name, cells in columns.items() if any("," in cell for cell in cells)
     }  # fmt: skip
     sure = any(found for found, _ in commas.values())
-    for (name, cells), unit in zip(columns.items(), units, strict=True):
+    for name, cells in columns.items():
         values, gaps, origin = numbers(cells, comma=True)
         if not gaps.text and (gaps.strange or name in commas):
             fault = ambiguity(cells, spelled)
@@ -212,7 +217,7 @@ def text_table(path: Path) -> Table:
             table.add_clock(name, times[0])
             table.notes.append(f"column {name!r} holds {times[1]}")
             continue
-        table.units[name] = unit
+        table.units[name] = told_units[name]
         table.add(name, values, gaps, origin, exact_of(cells, gaps))
     for clock, (first, counts) in dates.in_two_parts(table.columns).items():
         table.add_clock(clock, counts)

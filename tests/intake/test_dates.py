@@ -101,6 +101,22 @@ def test_a_clock_in_two_columns_is_one(tmp_path: Path) -> None:
     assert clock.back == 0
 
 
+def test_dates_and_times_of_day_in_two_columns_are_one_clock(tmp_path: Path) -> None:
+    stamps = ["2025-02-28,23:59:59.98", "2025-03-01,0:00:00.00", ",0:00:00.02"]
+    path = log(tmp_path, table("Date,Time,v", stamps))
+    found = read_log(path)
+    assert "columns 'Date' and 'Time' are one clock 'Time'" in found.notes[0]
+    assert list(found.columns) == ["Time", "v"] and np.isnan(found["Time"][2])
+    assert found["Time"][1] - found["Time"][0] == 20_000_000.0
+    assert inspect(path).topics[0].clock.began().startswith("2025-02-28 23:59:59.98")
+
+
+@pytest.mark.parametrize("rows", [["2025-03-01,left", "2025-03-01,right"], ["left,9:00:00"] * 2])
+def test_a_date_or_a_time_beside_other_texts_stays_alone(tmp_path: Path, rows: list[str]) -> None:
+    found = read_log(log(tmp_path, table("a,b,v", rows)))
+    assert not any("one clock" in note for note in found.notes)
+
+
 @pytest.mark.parametrize(
     "rows", ["1.5,3,0\n2.5,4,1\n", "1,2000000000,0\n2,0,1\n", "1,-5,0\n2,3,1\n"]
 )
