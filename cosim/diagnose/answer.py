@@ -69,6 +69,8 @@ class Verdict:
         others: laws of these that the named set has not, by rival.
         replaced: laws of the named set that the rival does without, by rival.
         places: named law -> other places (or laws) with which it would do the same.
+        alike: sets that the data do not tell from the named one, by their places in the table:
+            rivals, and those with a law of it elsewhere.
         left: channels above their noise, worst first.
         hints: nearest sets, of `unexplained`.
         force: the free force that explains most of the rest.
@@ -88,6 +90,7 @@ class Verdict:
     others: tuple[tuple[str, ...], ...] = ()
     replaced: tuple[tuple[str, ...], ...] = ()
     places: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    alike: tuple[int, ...] = ()
     left: tuple[Left, ...] = ()
     hints: tuple[Hint, ...] = ()
     force: Force | None = None

@@ -20,6 +20,7 @@ from ..calibrate.problem import Problem
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .adding import made_of
+from .alike import hold_all
 from .anew import asked_anew
 from .answer import Verdict
 from .bounds import opened, told
@@ -386,6 +387,8 @@ def _completed(result: Diagnosis, search: Search, current: Fitted, wide: list[Es
     after, answer = result.after, result.answer
     assert after is not None
     widen(search, after, wide)
+    others = [search.memo.get(result.table.models[i].labels) for i in answer.alike]
+    result.warnings += hold_all(after, [other for other in others if other is not None])
     result.small = small_laws(search, after)
     result.warnings += [law.sentence for law in result.small]
     if answer.rivals:

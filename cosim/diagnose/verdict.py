@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
+from .alike import held_by_all
 from .answer import Hint, Verdict, over, past, percent
 from .candidates import DELAY, LOG
 from .facts import Force, Gain, Law, Left, Model, Table, one_law
@@ -402,6 +403,7 @@ def _named(table: Table, best: int) -> Verdict:
         law.label: [t for t in law.twins if t not in _fitted(table)] for law in model.laws
     }
     rivals: list[tuple[int, float]] = []
+    alike: list[int] = []
     others: list[tuple[str, ...]] = []
     replaced: list[tuple[str, ...]] = []
     for i, rival in enumerate(table.models):
@@ -418,7 +420,9 @@ def _named(table: Table, best: int) -> Verdict:
             continue  # else a smaller set
         if len(mine) == len(other) == 1 and mine[0].effect == other[0].effect:
             places[mine[0].label].append(other[0].place)
+            alike.append(i)
         elif not _one_answer(model, rival):
+            alike.append(i)
             labels = tuple(law.label for law in other)
             same = [t for law in other[:1] if not other[1:] for t in law.twins
                     if t not in _fitted(table)]  # fmt: skip
@@ -436,13 +440,14 @@ def _named(table: Table, best: int) -> Verdict:
     return Verdict(
         "confounded" if rivals else "effect_found",
         best,
-        model.laws,
+        tuple(held_by_all(law, [table.models[i] for i in alike]) for law in model.laws),
         _explained(table, model, declared),
         shares,
         tuple(rivals[k] for k in order),
         tuple(others[k] for k in order),
         tuple(replaced[k] for k in order),
         {label: tuple(sorted(found)) for label, found in places.items() if found},
+        tuple(alike),
         _left(table, model),
         force=model.forces[0] if model.forces else None,
         ended=table.ended,
