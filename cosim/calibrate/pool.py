@@ -73,7 +73,8 @@ class SessionPool:
         budget: how much may be simulated; no limit if not given.
 
     Attributes:
-        outlines: the newest one of each run, whose table of inputs the next session shares.
+        outlines: the oldest one of each run that is still in use, whose table of inputs the next
+            session shares.
     """
 
     def __init__(self, budget: Budget | None = None) -> None:

@@ -97,7 +97,7 @@ class Simulator:
         master, duration, options = self._planned(run)
         place = (self._key(run).run, self.problem.step)
         session = Session(master, duration, like=self._pool.outlines.get(place), **options)
-        self._pool.outlines[place] = session.outline
+        self._pool.outlines.setdefault(place, session.outline)
         return session
 
     def session(self, run: MeasuredRun) -> Session:
