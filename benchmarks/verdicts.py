@@ -14,8 +14,9 @@ import argparse
 import json
 from pathlib import Path
 
+from cosim.diagnose.doubts import doubts
 from cosim.diagnose.facts import Table
-from cosim.diagnose.verdict import above, decide, doubts, stands
+from cosim.diagnose.verdict import above, decide, stands
 
 
 def main() -> None:

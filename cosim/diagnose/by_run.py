@@ -21,13 +21,14 @@ from ..calibrate.parts import Parameter
 from ..calibrate.simulator import Simulator
 from ..errors import CosimError
 from .answer import over, percent
+from .doubts import threshold
 from .facts import Left, Value
 from .linear import Absorber
 from .models import GATE_Z, Fitted, compare, value_of
 from .search import Search
 from .table import left_of
 from .values import Values, exact
-from .verdict import HALF, TENTH, above_noise, threshold
+from .verdict import HALF, TENTH, above_noise
 
 Vector = NDArray[np.float64]
 CLOSE = 0.9

@@ -13,12 +13,13 @@ import numpy as np
 from ..errors import CosimError
 from .candidates import Candidate
 from .composed import composed
+from .doubts import wanted
 from .late_values import LateValueFitter
 from .models import GATE, Fitted, compare
 from .redundant import at_usual, without_redundant
 from .rivals import challenged
 from .rounds import Round
-from .verdict import HAIR, TENTH, wanted
+from .verdict import HAIR, TENTH
 
 PART = 0.2
 """Share of what a model leaves beyond noise that a further effect must explain where runs may turn

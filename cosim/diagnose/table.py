@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from ..calibrate.foretelling import within_intervals
 from .bounds import beyond
+from .doubts import doubts, threshold
 from .facts import Comparison, Force, Law, Left, Model, Table, Value
 from .judge import Judge
 from .linear import BAND
 from .localise import Place, worst
 from .models import Fitted
 from .rounds import Round
-from .verdict import above, doubts, threshold, with_small
+from .verdict import above, with_small
 from .whiteness import whiteness_tests
 
 Vector = NDArray[np.float64]

@@ -15,17 +15,16 @@ Sentence, tables and JSON are written from the same facts: `answer.Verdict`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 
 from .alike import held_by_all
-from .answer import Hint, Verdict, over, past, percent
-from .candidates import DELAY, LOG
-from .facts import Force, Gain, Law, Left, Model, Table, one_law
+from .answer import Hint, Verdict, over, percent
+from .doubts import doubts, of_ticks, threshold, wanted
+from .facts import Force, Law, Left, Model, Table, one_law
 from .linear import MATERIAL
-from .models import GATE_Z, LEVEL
+from .models import GATE_Z
 from .whiteness import CALIBRATED, slowly
 
 FITTED = "identification"
@@ -43,15 +42,6 @@ that stick end that far from their minima."""
 HINTS, LEAST = 3, 0.01
 """Nearest sets that are listed, and the share of the excess that a hint must explain: what does not
 show in the percentage that is printed helps nobody."""
-
-
-def threshold(candidates: int) -> float:
-    """Log likelihood that unused runs must gain where there were so many candidates [nats].
-
-    The likelihood ratio of two fixed models has mean 1 if the simpler one is true, so for any of
-    N candidates it exceeds N / LEVEL with at most the probability LEVEL (Markov).
-    """
-    return math.log(max(candidates, 1) / LEVEL)
 
 
 def decide(table: Table) -> Verdict:
@@ -83,7 +73,10 @@ def proposal(table: Table) -> int | None:
     fewer that the data do not tell from them: two sensors that are late by as much are one late
     command.
     """
-    able = [i for i, model in enumerate(table.models) if not doubts(table, model)]
+    able = [
+        i for i, model in enumerate(table.models)
+        if not doubts(table, model) and not _of_ticks(table, i)
+    ]  # fmt: skip
     if not able:
         return None
     best = max(able, key=lambda i: (table.models[i].score, sorted(table.models[i].labels)))
@@ -103,6 +96,19 @@ def proposal(table: Table) -> int | None:
         alike = [i for i in able if i == best or not _apart(table, best, i)]
 
 
+def _of_ticks(table: Table, place: int) -> bool:
+    """Whether a set imitates one whose laws shift less than a tick, which does clearly better."""
+    model = table.models[place]
+    for i, rival in enumerate(table.models):
+        mine, other = _differ(model, rival)
+        if (
+            mine and other and len(rival.laws) <= len(model.laws) and of_ticks(table, rival)
+            and not _one_answer(model, rival) and _better(table, place, i)
+        ):  # fmt: skip
+            return True
+    return False
+
+
 def unasked(table: Table, best: int) -> list[int]:
     """Sets that would be the answer in the place of one if each of their laws is missed.
 
@@ -119,59 +125,6 @@ def unasked(table: Table, best: int) -> list[int]:
         and all(law.there for law in model.laws)
         and any(law.missed is None for law in model.laws)
     ]
-
-
-def doubts(table: Table, model: Model) -> list[str]:
-    """Why a set cannot be named whatever it leaves; nothing for one that can."""
-    if not model.laws:
-        return ["it is the declared model"]
-    found = []
-    if model.rough:
-        found.append("it was not worth a fit")
-    elif not table.unused_count:
-        found.append("no run was kept unused to judge by")
-    elif not wanted(model.gain, table.candidates):
-        gain, z = (model.gain.unused, model.gain.unused_z) if model.gain else (0.0, 0.0)
-        found.append(
-            f"unused runs do not want it ({gain:.3g} nats by {z:.2g} standard deviations; "
-            f"{threshold(table.candidates):.3g} by {GATE_Z:g} are needed)"
-        )
-    elif model.beyond is not None and not wanted(model.beyond, table.candidates):
-        found.append(f"the declared model does no worse with {past(table.bounds)}")
-    late = {law.label for law in model.laws if (law.component, law.effect) == (LOG, DELAY)}
-    if 0 < table.columns <= len(late):
-        found.append("it delays every column of the log, which is no delay of any")
-    for law in model.laws:
-        if not law.there:
-            edge = max(law.absent, law.size.minimum)
-            found.append(f"the interval of {law.label}'s {law.strength} holds {edge:g}: absence")
-        if abs(law.size.value) < law.tick:
-            found.append(f"{law.label} shifts nothing by a tick of the rig")
-        if model.rough or not table.unused_count:
-            continue
-        if law.missed is None:
-            found.append(f"what it is without {law.label} was not asked")
-        elif not wanted(law.missed, table.candidates):
-            if len(model.laws) > 1:
-                found.append(f"unused runs do not miss {law.label} if it is left out")
-        elif law.missed.change <= MATERIAL:
-            found.append(f"{law.label} changes no channel by {MATERIAL:g} of its noise")
-    return list(dict.fromkeys(found))
-
-
-def wanted(gain: Gain | None, candidates: int) -> bool:
-    """Whether unused runs want the better one of two models, and fitted runs do not speak against.
-
-    Args:
-        gain: of one over the other.
-        candidates: number of laws that there were to choose from.
-    """
-    return (
-        gain is not None
-        and gain.unused > threshold(candidates)
-        and gain.unused_z > GATE_Z
-        and gain.fitted > 0.0
-    )
 
 
 def above(model: Model) -> tuple[Left, ...]:

@@ -117,3 +117,36 @@ def test_what_is_told_to_be_detectable_was_simulated_about_as_weak(tmp_path: Pat
         rig.search.known = [rig.candidate(e) for e in ("coulomb", "viscous")]
         corrected = rig.search.scored(rig.base).corrected
     assert corrected[friction] < LEVEL < corrected[viscosity]
+
+
+@pytest.mark.parametrize(
+    ("late", "more", "kind"),
+    [
+        (3e-4, 40.0, "nothing_missing"),  # read within a tick; the other law imitates that
+        (3e-4, 5.0, "effect_found"),  # no better: the other law may be there
+        (6e-4, 40.0, "effect_found"),  # a law itself
+        (3e-4, -500.0, "effect_found"),  # small beside the other law
+    ],
+)
+def test_what_imitates_a_shift_within_a_tick_has_no_name(
+    late: float, more: float, kind: str
+) -> None:
+    """A wheel's speed is read 0.3 ms late, which a clock that loses 0.5 ms in a run nearly does."""
+    skew = law("clock_skew", "log.speed", value=2e-5, half=2e-6, gain=60.0, tick=1.5e-5)
+    shift = law("delay", "log.speed", value=late, half=1e-4, gain=60.0 + more, tick=5e-4)
+    sets = model(skew, gain=60.0), model(shift, gain=60.0 + more)
+    found = decide(table(model(), *sets))
+    assert found.kind == kind
+    if kind == "effect_found":
+        assert [x.effect for x in found.laws] == ["delay" if late > 5e-4 else "clock_skew"]
+
+
+@pytest.mark.parametrize("real", [True, False])
+def test_beside_a_law_a_shift_within_a_tick_takes_no_name_from_it(real: bool) -> None:
+    friction = law("coulomb", "motor.shaft")
+    skew = law("clock_skew", "log.speed", value=2e-5, half=2e-6, gain=60.0, tick=1.5e-5)
+    shift = law("delay", "log.speed", value=3e-4, half=1e-4, gain=100.0, tick=5e-4)
+    sets = model(friction), model(friction, skew, gain=60.0), model(friction, shift, gain=140.0)
+    found = decide(table(FAR, *(sets if real else sets[:2])))
+    assert found.kind == "effect_found"
+    assert [x.effect for x in found.laws] == ["coulomb", *(["clock_skew"] if not real else [])]

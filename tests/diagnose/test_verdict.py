@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from cosim.diagnose.answer import Verdict
+from cosim.diagnose.doubts import threshold
 from cosim.diagnose.facts import Comparison, Force, Gain, Law, Left, Model, Table, Value
 from cosim.diagnose.table import comparable
-from cosim.diagnose.verdict import above, beaten, decide, proposal, threshold, unasked
+from cosim.diagnose.verdict import above, beaten, decide, proposal, unasked
 
 COUNT = 4000
 """Measured values in identification runs, and in unused ones."""
